@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from ...physics.contact import Bank
 from ...physics.effects.base import Effect, Sensor
@@ -16,23 +17,29 @@ from ...physics.model import Block, LoadPoint, Model, Weakening
 from ...system.trace_cache import Program, of_this_package
 from .composition import DAMPING, PULL, SCALE
 from .force_along_motion import Way, along, as_sensed, lead, of_spring_force
-from .point import OWN
+from .point import LOCAL, OWN
 
 PROGRAMS = 64  # compiled at a time: each takes some two hundred mappings of memory, of which a process has 65530
 EMPTY = 1e-30  # N; an element that holds nothing still shows what it would do
+SHAPE = LOCAL.index("shape")
+VALUES = np.array([i for i in range(OWN) if i != SHAPE])  # of what is an event's own, those that are given at knots
 
 
 class Own(NamedTuple):
     """What differs from event to event in one run.
 
     Attributes:
-        value: of every event, in the order of :data:`LOCAL`, shape (e, 4); the last row is of none, and zero.
-        moves: 1 for an event, else 0, shape (e,).
-        of: at each knot the event of each, shape (n, 4).
+        value: of every knot's event, in the order of :data:`LOCAL` without the shape, shape (n, 3); zero where none is.
+        moves: 1 at a knot of an event, else 0, shape (n, 3).
+        shape: of every event; the last one stands for none, and is zero, shape (e,).
+        shapes: 1 for an event, else 0, shape (e,).
+        of: event of each knot, shape (n,).
     """
 
     value: Any
     moves: Any
+    shape: Any
+    shapes: Any
     of: Any
 
 
@@ -80,7 +87,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
     """
     a, b = len(names), len(phases)
 
-    def forces(z: Any, turn: Any, event: Any, scales: Any, fixed: Any, common: CommonInput, run: RunInput) -> Any:
+    def forces(z: Any, turn: Any, own: Own, scales: Any, fixed: Any, common: CommonInput, run: RunInput) -> Any:
         effects, way, knots = jax.tree.unflatten(structure, common.effects), run.way, run.knots
         si = {n: jnp.where(s == 0.0, jnp.exp(v), v * s) for n, v, s in zip(names, z, scales, strict=True)}
         values = {**fixed, **si, **dict(zip(phases, turn, strict=True))}
@@ -102,7 +109,7 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         if way.force_scale is not None:
             seen = of_spring_force(model, seen, values[SCALE])
         shift = seen.x - way.x
-        held = along(model, of_events(seen, event, run.own.of), knots)
+        held = along(model, of_events(seen, own), knots)
         led = lead(model, way.t, way.drive)
         steep = jax.vmap(jax.grad(model.pull))(led - seen.x)
         # what a reading counts for: by the force of the spring, and by the displacement
@@ -119,12 +126,13 @@ def compiled(names: tuple[str, ...], phases: tuple[str, ...], structure: Any, wh
         own = run.own
 
         def moved(row: Any) -> Any:
-            def f(z: Any, turn: Any, event: Any) -> Any:
-                return forces(z, turn, event, scales, fixed, common, run)
+            def f(z: Any, turn: Any, value: Any, shape: Any) -> Any:
+                return forces(z, turn, own._replace(value=value, shape=shape), scales, fixed, common, run)
 
             # all events are moved at once: each acts on its own points only
-            step = own.moves[:, None] * row[a + b :]
-            return jax.jvp(f, (z, turn, own.value), (row[:a], row[a : a + b] * turn_scale, step), has_aux=True)
+            steps = own.moves * row[a + b :][VALUES], own.shapes * row[a + b + SHAPE]
+            given = (z, turn, own.value, own.shape), (row[:a], row[a : a + b] * turn_scale, *steps)
+            return jax.jvp(f, *given, has_aux=True)
 
         out, slope, aux = jax.vmap(moved, out_axes=(None, 0, None))(jnp.eye(a + b + OWN)[0 if whole else a + b :])
         return *out, *slope, *aux
@@ -154,13 +162,13 @@ def _set(effect: Effect, values: dict[str, Any]) -> Effect:
     return effect
 
 
-def of_events(way: Way, event: Any, of: Any) -> Way:
-    """The way with what differs from event to event, shapes (e, 4) and (n, 4)."""
-    strength, stretch, _, offset = (event[of[:, i], i] for i in range(OWN))
+def of_events(way: Way, own: Own) -> Way:
+    """The way with what differs from event to event."""
+    strength, stretch, offset = own.value.T
     return way._replace(
         x=way.x + offset,
         strength=way.strength * jnp.exp(strength),
         stretch=way.stretch * jnp.exp(stretch),
-        shape=event[:, 2],
-        of=of[:, 2],
+        shape=own.shape,
+        of=own.of,
     )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...physics.effects.base import Sensor
 from ...system.threads import side_by_side
 from ..fit.parameters import to_si
-from .compiled_force import EMPTY, CommonInput, Own, RunInput, compiled
+from .compiled_force import EMPTY, SHAPE, VALUES, CommonInput, Own, RunInput, compiled
 from .composition import BESIDE, DAMPING, Composition
 from .force_along_motion import Way
 from .knots import PHASES, Knots
@@ -263,10 +263,10 @@ class Problem:
     def own(self, point: Point) -> list[Own]:
         """What differs from event to event in every run."""
         out = []
-        for first, run, own in zip(self.first, self.runs, self._own, strict=True):
-            value = np.zeros(own.value.shape)
+        for first, run, (own, of) in zip(self.first, self.runs, self._own, strict=True):
+            value = np.zeros((own.shape.size, OWN))
             value[: run.events] = point.events[first : first + run.events]
-            out.append(own._replace(value=value))
+            out.append(own._replace(value=value[of, VALUES], shape=value[:, SHAPE]))
         return out
 
     def common_input(self, point: Point) -> CommonInput:
@@ -453,9 +453,13 @@ def _hats(place: Array) -> Array:
     return np.stack([np.interp(place, NODES, row) for row in np.eye(len(NODES))], axis=1)
 
 
-def _own(k: Knots, n: int, most: int) -> Own:
-    """Of each knot the event of each of :data:`LOCAL`; the last one of all stands for none."""
+def _own(k: Knots, n: int, most: int) -> tuple[Own, NDArray[np.intp]]:
+    """What may differ from event to event, all of it zero, and of each knot the event of each of :data:`VALUES`.
+
+    The last event of all stands for none.
+    """
     of = np.full((n, OWN), most - 1)
     for column, event in enumerate((k.event, k.event, k.event, k.arrest)):
         of[: k.t.size, column] = np.where((event >= 0) & (event < k.events), event, most - 1)
-    return Own(np.zeros((most, OWN)), (np.arange(most) < k.events).astype(float), of)
+    shapes, at = (np.arange(most) < k.events).astype(float), of[:, VALUES]
+    return Own(np.zeros(at.shape), shapes[at], np.zeros(most), shapes, of[:, SHAPE]), at

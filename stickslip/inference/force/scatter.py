@@ -42,7 +42,8 @@ NUMERIC = 1e-4  # share of the strength below which nothing is claimed
 REACH = 1.0  # correlation length along the place
 FARTHEST = 1.5  # step of a size, in e-folds
 DAMPINGS = 6  # of a step that does not lower the cost
-SETTLED = 0.05  # fall of the cost at which the search ends
+LEAST = 1e-2  # damping of a step, over the second derivative
+SETTLED = 0.05  # fall of the cost, expected or found, at which the search ends
 EXACT = 0.02  # of a level, to which any process describes it
 PARTS = ("both", "static", "sliding")  # of friction, that wander
 SHORTEST = 2.0  # length of a wander, in usual distances of events: it goes on from one to the next
@@ -382,7 +383,7 @@ def weigh(sizes: Array, residual: Array, k: Known, root: Array | None = None) ->
 
 
 def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
-    """Gradient of the cost and its average information, one for each size."""
+    """Gradient of the cost, one for each size, and what stands for its second derivative (see :func:`estimate`)."""
     s = np.exp(sizes)
     found = weigh(sizes, residual, k, root)
     a, inverted = found.weighted, found.inverted
@@ -425,15 +426,19 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
     centres, widths = k.expected
+    second = 2.0 * np.maximum(gradient, 0.0)
+    if k.chain is not None:
+        second[_LENGTH] = 0.0
     gradient += 2.0 * (sizes - centres) / widths**2
-    return gradient, information + np.diag(2.0 / widths**2)
+    return gradient, information + np.diag(second + 2.0 / widths**2)
 
 
 def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> Scatter:
     """The sizes under which residuals (E, n), random effects at zero, are most likely.
 
-    Newton's method with the average information (Gilmour, Thompson & Cullis 1995) in place of the second derivative,
-    damped, within bounds around what is expected.
+    Newton's method, damped, within bounds around what is expected. In place of the second derivative it has the average
+    information (Gilmour, Thompson & Cullis 1995) and, as the covariance goes with the square of each size, twice the
+    gradient where that is positive: sizes that only what is expected of them holds up would be overshot otherwise.
 
     Raises:
         FitError: the covariance is not positive definite in double precision.
@@ -447,7 +452,7 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     if known.chain is not None:  # shorter ones are no wander, and longer ones would be a level of every run
         low[_LENGTH], high[_LENGTH] = np.log(SHORTEST), np.log(max(known.chain.longest, 2.0 * SHORTEST))
         high[_BEND] = 0.0
-    sizes, damping = np.clip(start.sizes, low, high), 1e-2
+    sizes, damping = np.clip(start.sizes, low, high), LEAST
     cost, root = _misfit(sizes, residual, known)
     if not np.isfinite(cost):
         raise FitError("the model's forces differ so much from event to event that no likelihood can be given")
@@ -460,9 +465,12 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
             step = np.zeros(sizes.size)
             step[free] = -np.linalg.solve(matrix, gradient[free])
             trial = np.clip(sizes + np.clip(step, -FARTHEST, FARTHEST), low, high)
+            change = trial - sizes
+            if -(gradient + 0.5 * information @ change) @ change < SETTLED:
+                break
             there, other = _misfit(trial, residual, known)
             if there < cost:
-                fallen, cost, sizes, root, damping = cost - there, there, trial, other, max(0.1 * damping, 1e-6)
+                fallen, cost, sizes, root, damping = cost - there, there, trial, other, max(0.1 * damping, LEAST)
                 break
             damping *= 10.0
         if fallen < SETTLED:

@@ -96,7 +96,7 @@ def _program(base: Any, structure: Any, cls: type[Effect]) -> Program:
             if PULL in everything:
                 moving = moving._replace(drive=moving.drive + everything[PULL] / model.block.spring_stiffness)
             seen = of_block(model, moving, everything.get(SCALE, 1.0), knots)
-            held = along(model, of_events(seen, run.own.value, run.own.of), knots)
+            held = along(model, of_events(seen, run.own), knots)
             return held.pull + held.body - held.contact, seen.x - way.x, model.mass()
 
         return jax.jvp(forces, (values[names[place]],), (jnp.ones(()),))[1]
