@@ -383,7 +383,7 @@ def weigh(sizes: Array, residual: Array, k: Known, root: Array | None = None) ->
 
 
 def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
-    """Gradient of the cost, one for each size, and what stands for its second derivative (see :func:`estimate`)."""
+    """Gradient of the cost and its average information, one for each size."""
     s = np.exp(sizes)
     found = weigh(sizes, residual, k, root)
     a, inverted = found.weighted, found.inverted
@@ -426,11 +426,8 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
     centres, widths = k.expected
-    second = 2.0 * np.maximum(gradient, 0.0)
-    if k.chain is not None:
-        second[_LENGTH] = 0.0
     gradient += 2.0 * (sizes - centres) / widths**2
-    return gradient, information + np.diag(second + 2.0 / widths**2)
+    return gradient, information + np.diag(2.0 / widths**2)
 
 
 def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> Scatter:
@@ -458,6 +455,10 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
         raise FitError("the model's forces differ so much from event to event that no likelihood can be given")
     for _ in range(steps):
         gradient, information = _slopes(sizes, residual, known, root)
+        by_square = 2.0 * (gradient - 2.0 * (sizes - centres) / widths**2)
+        if known.chain is not None:
+            by_square[_LENGTH] = 0.0
+        information += np.diag(np.maximum(by_square, 0.0))
         free = ~(((sizes <= low) & (gradient > 0.0)) | ((sizes >= high) & (gradient < 0.0)))
         fallen = 0.0
         for _ in range(DAMPINGS):
