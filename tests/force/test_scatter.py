@@ -157,7 +157,7 @@ def test_sizes_are_found_in_what_was_drawn_from_them():
     for seed in range(20, 32):
         residual = drawn(true(), known, seed)
         sizes = estimate(Scatter.wide(), residual, known, steps=200).sizes
-        _, information = _slopes(sizes, residual, known, _misfit(sizes, residual, known)[1])
+        _, information, _ = _slopes(sizes, residual, known, _misfit(sizes, residual, known)[1])
         sd = np.sqrt(np.diag(2.0 * np.linalg.inv(information)))
         found.append((sizes - true()) / sd)
         stated.append(sd)
@@ -203,7 +203,7 @@ def test_slopes_are_those_of_the_cost():
     known = events(short=True)
     residual = np.random.default_rng(3).standard_normal((EVENTS, POINTS)) * 1e-3 * STRENGTH * known.there
     at = true() + 0.3
-    gradient, information = _slopes(at, residual, known, _misfit(at, residual, known)[1])
+    gradient, information, _ = _slopes(at, residual, known, _misfit(at, residual, known)[1])
     for step in (1e-3, 1e-4, 1e-5):
         seen = [
             (misfit(at + d, residual, known) - misfit(at - d, residual, known)) / (2 * step)

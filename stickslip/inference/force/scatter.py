@@ -382,8 +382,12 @@ def weigh(sizes: Array, residual: Array, k: Known, root: Array | None = None) ->
     return Weighed(inverted, weighted[..., 0], linked, stands[..., 0], back, residual[..., 0])
 
 
-def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array]:
-    """Gradient of the cost and its average information, one for each size."""
+def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array, Array, Array]:
+    """Gradient of the cost, its average information, and what the squares of the sizes add to it, one for each size.
+
+    The covariance goes with the square of a size, so that twice the gradient belongs to the second derivative, but for
+    the share that the size has of the covariance where it acts: of all of it the information holds that already.
+    """
     s = np.exp(sizes)
     found = weigh(sizes, residual, k, root)
     a, inverted = found.weighted, found.inverted
@@ -425,17 +429,22 @@ def _slopes(sizes: Array, residual: Array, k: Known, root: Array) -> tuple[Array
             moved[..., size] += power * part + np.einsum("eik,ek->ei", loads, of_states[k.chain.states])
     white = found.linked.apart(found.back @ moved).reshape(-1, sizes.size)
     information = white.T @ white
+    acts = 2.0 * np.einsum("ei,eis->s", a, moved)
+    share = np.divide(np.diag(information), acts, out=np.ones(sizes.size), where=acts > 0.0)
+    squares = 2.0 * gradient * np.clip(1.0 - share, 0.0, 1.0)
+    if k.chain is not None:
+        squares[_LENGTH] = 0.0
     centres, widths = k.expected
     gradient += 2.0 * (sizes - centres) / widths**2
-    return gradient, information + np.diag(2.0 / widths**2)
+    return gradient, information + np.diag(2.0 / widths**2), squares
 
 
 def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> Scatter:
     """The sizes under which residuals (E, n), random effects at zero, are most likely.
 
     Newton's method, damped, within bounds around what is expected. In place of the second derivative it has the average
-    information (Gilmour, Thompson & Cullis 1995) and, as the covariance goes with the square of each size, twice the
-    gradient where that is positive: sizes that only what is expected of them holds up would be overshot otherwise.
+    information (Gilmour, Thompson & Cullis 1995) and what squares add to it where that is positive: sizes that only
+    what is expected of them holds up would be overshot otherwise.
 
     Raises:
         FitError: the covariance is not positive definite in double precision.
@@ -454,11 +463,8 @@ def estimate(start: Scatter, residual: Array, known: Known, steps: int = 30) -> 
     if not np.isfinite(cost):
         raise FitError("the model's forces differ so much from event to event that no likelihood can be given")
     for _ in range(steps):
-        gradient, information = _slopes(sizes, residual, known, root)
-        by_square = 2.0 * (gradient - 2.0 * (sizes - centres) / widths**2)
-        if known.chain is not None:
-            by_square[_LENGTH] = 0.0
-        information += np.diag(np.maximum(by_square, 0.0))
+        gradient, information, squares = _slopes(sizes, residual, known, root)
+        information += np.diag(np.maximum(squares, 0.0))
         free = ~(((sizes <= low) & (gradient > 0.0)) | ((sizes >= high) & (gradient < 0.0)))
         fallen = 0.0
         for _ in range(DAMPINGS):
