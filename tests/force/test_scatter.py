@@ -182,21 +182,15 @@ def test_events_differ_no_more_than_they_may():
 
 
 @pytest.mark.parametrize("small", [(), ("stretch", "shape", "position"), ("walk", "fringe", "creep")])
-def test_a_search_for_sizes_ends_where_none_of_them_lowers_the_cost(small):
+def test_searches_for_sizes_from_anywhere_end_at_one_minimum(small):
     """Also for sizes that the residuals put at zero, where only what is expected of them holds them up."""
     known, sizes = events(short=True), true()
     for name in small:
         sizes[NAMES.index(name)] -= np.log(1e3)
     residual = drawn(sizes, known, 22)
-    at = estimate(Scatter.wide(), residual, known).sizes
-    least, d = misfit(at, residual, known), 0.1
-    for name, step in zip(NAMES, d * np.eye(len(NAMES)), strict=True):
-        if name == "white":  # which stands at its bound
-            continue
-        less, more = (misfit(at + side * step, residual, known) - least for side in (-1.0, 1.0))
-        slope, curvature = (more - less) / (2.0 * d), (more + less) / d**2
-        assert curvature > 0.0, name
-        assert slope**2 / (2.0 * curvature) < 0.05, (name, slope, curvature)
+    starts = (Scatter.wide(), *(Scatter(at) for at in (sizes, true(), true() + 1.0, true() - 1.0)))
+    costs = [misfit(estimate(start, residual, known).sizes, residual, known) for start in starts]
+    assert np.ptp(costs) < 0.1
 
 
 def test_slopes_are_those_of_the_cost():
