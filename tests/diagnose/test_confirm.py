@@ -119,7 +119,7 @@ def test_sliding_friction_that_differs_in_every_event_is_another_drop(plain):
     _, other, _ = simulated(m, base.problem, replace(base.point, z=z), 0, 0)
     _, as_fitted, _ = simulated(m, base.problem, base.point, 0, 0)
     np.testing.assert_allclose(found, other, rtol=1e-9, atol=1e-15)
-    assert np.abs(found - as_fitted).max() > 1e-3 * np.abs(as_fitted).max()
+    assert np.nanmax(np.abs(found / as_fitted - 1.0)) > 1e-2  # features differ in their units
 
 
 def test_wrong_parameters_show(stronger, confirmed):
