@@ -137,7 +137,7 @@ def test_slopes_are_those_of_the_cost(way):
     known = levelled(way)
     residual = np.random.default_rng(3).standard_normal((EVENTS, POINTS)) * 2.5e-4 * known.there
     at = sizes() + 0.3
-    gradient, information = _slopes(at, residual, known, _misfit(at, residual, known)[1])
+    gradient, information, _ = _slopes(at, residual, known, _misfit(at, residual, known)[1])
     seen = [(misfit(at + d, residual, known) - misfit(at - d, residual, known)) / 2e-4 for d in 1e-4 * np.eye(at.size)]
     np.testing.assert_allclose(gradient, seen, rtol=2e-4, atol=1e-5 * np.abs(gradient).max())
     # average information: the residuals' quadratic form in the derivatives of the dense covariance
@@ -163,7 +163,7 @@ def test_size_and_length_are_found_in_what_was_drawn_from_them():
     for seed in range(40, 64):
         residual = drawn(sizes(), known, seed)
         at = estimate(start, residual, known, steps=200).sizes
-        _, information = _slopes(at, residual, known, _misfit(at, residual, known)[1])
+        _, information, _ = _slopes(at, residual, known, _misfit(at, residual, known)[1])
         found.append(((at - sizes()) / np.sqrt(np.diag(2.0 * np.linalg.inv(information))))[-3:-1])
     mean, spread = np.mean(found, axis=0), np.std(found, axis=0)
     assert np.abs(mean).max() < 3.5 / np.sqrt(len(found)), (mean, spread)
