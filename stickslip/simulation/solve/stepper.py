@@ -11,9 +11,8 @@ where elements stick as the block slows down, is kept without landing on it.
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import diffrax
 import equinox as eqx
@@ -25,23 +24,23 @@ from jax import Array
 from ...physics.contact import Bank
 from ...physics.effects.base import Contact, Motion
 from ...physics.model import Forces, Model, State, Work
-from .oscillation import Oscillation
-from .tolerance import Tolerance
+from .oscillation import Oscillation, followed, widest
+from .stages import (
+    GAMMA,
+    D,
+    Stage,
+    first_stage,
+    integral,
+    integral_of_square,
+    local_error,
+    second_stage,
+    work_of_spring,
+)
+from .tolerance import TINY, Tolerance
 from .trajectory import hermite
 
-GAMMA = 2.0 - math.sqrt(2.0)
-D = GAMMA / 2.0  # weight of the implicit end point in both stages
-W = math.sqrt(2.0) / 4.0  # weight of the start and of the first stage in the second
-NEAR = 0.01
-HELD = 0.25
-WIDEST = (1.0, 2.0)
-VALUES = (0.2439339828220164, 0.49748737341529026, 0.2585786437626934)
-RATES = (0.01809644062711475, -0.048570226039552994, -0.01952621458756389)
-STEEP = (1.0, 4.0)
-KEPT, OVER = 0.53, 0.3
-
-# embedded third-order weights minus those of the method
-E0, E1, E2 = (1.0 - W) / 3.0 - W, (3.0 * W + 1.0) / 3.0 - W, D / 3.0 - D
+SHORT = 0.53  # error after which the controller keeps the length of the step
+UNHEARD = 0.3  # of the velocity's amplitude: at most the error of a step that does not follow the oscillation
 
 
 class Increments(diffrax.AbstractTerm):
@@ -131,27 +130,25 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         tol = self.tolerance
         dh = D * h
         exact = 1e-3 * tol.velocity + 1e-4 * tol.relative * jnp.abs(v0)
-        swing, share = _swing(model, bank, y0, contact, a0, t0, h)
+        swing, share = followed(model, bank, y0, contact, a0, t0, h)
 
-        def stage(t: Array, dt: Array, plan: Stage, guess: Array) -> tuple:
-            """Solve for the end velocity; the path runs from the start of the step."""
-            problem = (model, bank, y0, a0, contact, t, dt, plan, swing, model.lead(t))
+        def stage(t: Array, dt: Array, form: Stage, guess: Array) -> tuple:
+            """Solve for the velocity at the stage; the path runs from the start of the step."""
+            problem = (model, bank, y0, a0, contact, t, dt, form, swing, model.lead(t))
             v, slope, converged, (state, forces, motion) = _root(problem, guess, exact, self.newton_steps)
-            beyond = (v - plan.v) / plan.into_v
+            beyond = (v - form.v) / form.into_v
             a = a0 - swing.stiffness * motion.dx - swing.damping * (v - v0) + beyond
             return v, a, beyond, state, forces, motion, slope, converged
 
-        plan = _first_stage(swing, share, v0, a0, h)
-        v1, a1, n1, _, f1, m1, _, ok1 = stage(t0 + GAMMA * h, GAMMA * h, plan, v0)
-        plan = _second_stage(swing, share, (v0, v1), (a0, a1), n1, m1.dx, h)
-        v2, a2, n2, y1, f2, m2, slope, ok2 = stage(t1, h, plan, v1)
+        first = first_stage(swing, share, v0, a0, h)
+        v1, a1, n1, _, f1, m1, _, ok1 = stage(t0 + GAMMA * h, GAMMA * h, first, v0)
+        second = second_stage(swing, share, (v0, v1), (a0, a1), n1, h)
+        v2, a2, n2, y1, f2, m2, slope, ok2 = stage(t1, h, second, v1)
 
-        # of what comes on top of the oscillation, or of all
-        beyond = h * (E1 * n1 + E2 * n2)
-        ex = share * 0.5 * h * beyond + (1.0 - share) * h * (E0 * v0 + E1 * v1 + E2 * v2)
-        ev = share * beyond + (1.0 - share) * h * (E0 * a0 + E1 * a1 + E2 * a2)
-        whole = slope * (1.0 + dh * (swing.damping + dh * swing.stiffness))
-        slope = slope + (1.0 - share) * (whole - slope)
+        v, a = (v0, v1, v2), (a0, a1, a2)
+        ex, ev = local_error(v, a, (n1, n2), share, h)
+        whole = slope * (1.0 + dh * (swing.damping + dh * swing.stiffness))  # with the tangent of the oscillation
+        slope = whole + share * (slope - whole)
         # stiff part of the estimate damped by (1 - D h J)^-1, J the tangent of the second stage
         ex, ev = (ex + dh * ev) / slope, (ev - (slope - 1.0) / dh * ex) / slope
         sx = tol.displacement + tol.relative * m2.path
@@ -161,10 +158,11 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         ex = jnp.sqrt(ex**2 + ev**2 / (held + driving))
         rx, rv = tol.ring(v2, a0, a2, h, held, driving)
         sx, sv = sx + rx, sv + rv
-        # beyond the widest angle only what rings no more
-        angle, pace = swing.angle(h), jnp.sqrt(swing.stiffness) + 1e-30
-        rings = jnp.maximum(jnp.abs(a0), jnp.abs(a2)) / pace + jnp.abs(a2 - a0) / (h * pace**2)
-        ahead = jnp.minimum(KEPT * (angle / WIDEST[0]) ** 3, OVER * rings * jnp.maximum(1.0 / sv, 1.0 / (pace * sx)))
+        # no error would tell of a step so wide that it does not follow what it should
+        rate = jnp.sqrt(swing.stiffness) + TINY
+        rings = jnp.maximum(abs(a0), abs(a2)) / rate + abs(a2 - a0) / (h * rate**2)
+        missed = UNHEARD * rings * jnp.maximum(1.0 / sv, 1.0 / (rate * sx))
+        wide = jnp.where(share > 0.0, jnp.minimum(SHORT * (swing.angle(h) / widest(model)) ** 3, missed), 0.0)
         ok = ok1 & ok2
         error = jax.tree.map(jnp.zeros_like, y0)
         error = eqx.tree_at(
@@ -172,115 +170,19 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
             error,
             (
                 jnp.where(ok, ex / sx, jnp.inf),
-                jnp.where(ok, jnp.maximum(jnp.abs(ev) / sv, jnp.where(share > 0.0, ahead, 0.0)), jnp.inf),
+                jnp.where(ok, jnp.maximum(abs(ev) / sv, wide), jnp.inf),
             ),
         )
-        work = _work(y0, contact, (v0, v1, v2), (a0, a1, a2), (m1.dx, m2.dx), (f1, f2), h, share, model)
+        w, block = y0.work, model.block
+        pull, body = (contact.spring_force, f1.spring, f2.spring), (f1.body * v0, f1.body * v1, f2.body * v2)
+        work = Work(
+            w.spring + work_of_spring(pull, block.spring_stiffness, (m1.dx, m2.dx), v, a, share, h),
+            w.friction + f2.dissipated,
+            w.viscous + block.damping * integral_of_square(v, a, share, h),
+            w.body + integral(body, share, h) + f2.given,
+        )
         y1 = eqx.tree_at(lambda y: y.work, y1, work)
         return y1, error, {"y0": y0, "y1": y1}, Step(a2, ~ok), diffrax.RESULTS.successful
-
-
-class Stage(NamedTuple):
-    """A stage's end as a function of what acts beyond the oscillation there, ``n`` (m/s^2): ``dx + into_x n`` and
-    ``v + into_v n``."""
-
-    dx: Array
-    v: Array
-    into_x: Array
-    into_v: Array
-
-
-def _smooth(s: Array) -> Array:
-    """From 0 at 0 to 1 at 1 without an edge."""
-    s = jnp.clip(s, 0.0, 1.0)
-    return s * s * (3.0 - 2.0 * s)
-
-
-def _swing(model: Model, bank: Bank, y0: State, contact: Contact, a0: Array, t0: Array, h: Array) -> tuple[Oscillation, Array]:
-    """The oscillation of the block on all that holds it at the start of a step, and its share in the step, 0 ... 1.
-
-    An element counts as far as it does not slide on the way ahead. Both follow the state without a jump.
-    """
-    mass = model.mass()
-    driving, damping = model.block.spring_stiffness / mass, model.block.damping / mass
-    total = jnp.sum(y0.stiffness) / mass + 1e-300
-    square = (total + driving) * h * h
-    way = h * v_way(y0.v, square, 6.0) + 0.5 * h * h * v_way(a0, square, 12.0)
-    blur = NEAR * (jnp.abs(y0.v) * h + 0.5 * jnp.abs(a0) * h * h) + 1e-30
-    room = y0.cap - jnp.where(way < 0.0, -1.0, 1.0) * y0.force
-    ahead = 1.0 / (jnp.abs(way) + blur)
-    held = jnp.sum(jnp.minimum(y0.stiffness, (room + y0.stiffness * blur) * ahead)) / mass
-    swing = Oscillation(driving + held, damping)
-    zero = jnp.zeros(())
-    still = Motion(t0 + zero, zero + 1e-12, y0.x, zero + 1e-12, zero, zero, model.lead(t0))
-    steep = h / mass * model.velocity_slope(y0, bank, contact, still)
-    share = _smooth((held / total - HELD) / HELD) * _smooth(WIDEST[1] - swing.angle(h))
-    share = share * _smooth((STEEP[1] - steep) / (STEEP[1] - STEEP[0]))
-    return jax.tree.map(lambda a: jnp.where(share > 0.0, a, 0.0), swing), share
-
-
-def v_way(v, square, n):
-    return v / (1.0 + square / n)
-
-
-def _first_stage(swing: Oscillation, share: Array, v0: Array, a0: Array, h: Array) -> Stage:
-    d, t = D * h, GAMMA * h
-    k, c = swing.stiffness, swing.damping
-    into = d / (1.0 + d * (c + d * k))
-    gain = 2.0 * into * (a0 - d * k * v0)
-    plain = Stage(d * (2.0 * v0 + gain), v0 + gain, d * into, into)
-    r = swing.responses(t)
-    free = v0 * t + a0 * r.constant - k * v0 * r.linear, v0 + a0 * r.push - k * v0 * r.constant
-    exact = Stage(*free, r.linear / t, r.constant / t)
-    return Stage(*(a + share * (b - a) for a, b in zip(plain, exact, strict=True)))
-
-
-def _second_stage(swing, share, v, a, n1, dx1, h):
-    d, t = D * h, GAMMA * h
-    k, c = swing.stiffness, swing.damping
-    into = d / (1.0 + d * (c + d * k))
-    dx, dv = W * h * (v[0] + v[1]), W * h * (a[0] + a[1])
-    gain = (dv + d * (a[0] - k * (dx + d * v[0]))) / (1.0 + d * (c + d * k))
-    plain = Stage(dx + d * (v[0] + gain), v[0] + gain, d * into, into)
-    r = swing.responses(h)
-    free = v[0] * h + a[0] * r.constant - k * v[0] * r.linear, v[0] + a[0] * r.push - k * v[0] * r.constant
-    curve = 2.0 / (h * (h - t))  # of the parabola through zero at the start and at the first stage, one at the end
-    curve1 = -2.0 / (t * (h - t))
-    rise, rise1 = -0.5 * t * curve, 1.0 / t - 0.5 * t * curve1
-    exact = Stage(
-        free[0] + n1 * (rise1 * r.linear + curve1 * r.quadratic),
-        free[1] + n1 * (rise1 * r.constant + curve1 * r.linear),
-        rise * r.linear + curve * r.quadratic,
-        rise * r.constant + curve * r.linear,
-    )
-    return Stage(*(a + share * (b - a) for a, b in zip(plain, exact, strict=True)))
-
-
-def _work(y0: State, contact: Contact, v, a, dx, f: tuple, h: Array, share, model: Model) -> Work:
-    """Energies of the step: by the weights of the stages, or with the course of the oscillation between them."""
-    v0, v1, v2 = v
-    f1, f2 = f
-    w, c, pull = y0.work, model.block.damping, contact.spring_force
-
-    def quadrature(p0: Array, p1: Array, p2: Array) -> Array:
-        exact = W + share * E0, W + share * E1, D + share * E2
-        return h * (exact[0] * p0 + exact[1] * p1 + exact[2] * p2)
-
-    # what the spring's force is without the block's displacement is smooth: a parabola
-    c_s, (dx1, dx2) = model.block.spring_stiffness, dx
-    rise1, rise2 = f1.spring - pull + c_s * dx1, f2.spring - pull + c_s * dx2
-    curve = (rise1 / GAMMA - rise2) / (GAMMA - 1.0)
-    dv, da = h * v0, h * h * a[0]
-    mean = 0.5 * dx2 + 0.1 * h * (v0 - v2) + h * h * (a[0] + a[2]) / 120.0
-    first = (75.0 * dx2 + 8.0 * dv - 13.0 * h * v2) / 210.0 + da / 280.0 + h * h * a[2] / 210.0
-    swung = pull * dx2 - 0.5 * c_s * dx2**2 + (rise2 - curve) * (dx2 - mean) + curve * (dx2 - 2.0 * first)
-    spring = quadrature(pull * v0, f1.spring * v1, f2.spring * v2)
-    plain = quadrature(v0 * v0, v1 * v1, v2 * v2)
-    rates = sum(q * p * r for q, p, r in zip(RATES, v, a, strict=True))
-    smooth = h * (sum(q * p * p for q, p in zip(VALUES, v, strict=True)) + 2.0 * h * rates)
-    body = quadrature(f1.body * v0, f1.body * v1, f2.body * v2)
-    spring, square = spring + share * (swung - spring), plain + share * (smooth - plain)
-    return Work(w.spring + spring, w.friction + f2.dissipated, w.viscous + c * square, w.body + body + f2.given)
 
 
 def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: Array) -> Motion:
@@ -298,16 +200,16 @@ def _increment(
     contact: Contact,
     t: Array,
     dt: Array,
-    plan: Stage,
+    form: Stage,
     swing: Oscillation,
     lead: Array,
 ) -> tuple[Array, tuple[State, Forces, Motion]]:
     """Residual of a stage's equation for the end velocity ``v``, and what the increment then leads to."""
-    dx = plan.dx + plan.into_x / plan.into_v * (v - plan.v)
+    dx = form.dx + form.into_dx / form.into_v * (v - form.v)
     motion = _path(t, dt, y0.x, y0.v, v, dx, lead)
     state, forces = model.advance(y0, bank, contact, motion)
     beyond = forces.net / model.mass() - a0 + swing.stiffness * dx + swing.damping * (v - y0.v)
-    return v - plan.v - plan.into_v * beyond, (state, forces, motion)
+    return v - form.v - form.into_v * beyond, (state, forces, motion)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
