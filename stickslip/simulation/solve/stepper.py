@@ -4,8 +4,9 @@ A vector field with kinks handed to a stock solver is an invalid input: the kink
 stops to slide. Here a step is an increment, as in finite elements: position and velocity follow TR-BDF2 (Bank et al.
 1985; L-stable, second order, third-order error estimate of Hosea & Shampine 1996), while contact and effects are
 taken by their own exact or implicit update from the start of the step to each of its two stages. Each stage is a
-scalar equation in the velocity, solved by Newton's method. The path of a step is a parabola: where it turns, and
-where elements stick as the block slows down, is kept without landing on it.
+scalar equation in the velocity, solved by Newton's method. Where the contact holds the block the stages follow its
+oscillation in closed form (:mod:`.stages`). The path of a step is a parabola: where it turns, and where elements stick
+as the block slows down, is kept without landing on it.
 """
 
 from __future__ import annotations
