@@ -142,9 +142,10 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
             return v, a, beyond, state, forces, motion, slope, converged
 
         first = first_stage(swing, share, v0, a0, h)
-        v1, a1, n1, _, f1, m1, _, ok1 = stage(t0 + GAMMA * h, GAMMA * h, first, v0)
+        v1, a1, n1, _, f1, m1, _, ok1 = stage(t0 + GAMMA * h, GAMMA * h, first, v0 + share * (first.v - v0))
         second = second_stage(swing, share, (v0, v1), (a0, a1), n1, h)
-        v2, a2, n2, y1, f2, m2, slope, ok2 = stage(t1, h, second, v1)
+        guess = second.v + second.into_v * n1 / GAMMA
+        v2, a2, n2, y1, f2, m2, slope, ok2 = stage(t1, h, second, v1 + share * (guess - v1))
 
         v, a = (v0, v1, v2), (a0, a1, a2)
         ex, ev = local_error(v, a, (n1, n2), share, h)
