@@ -18,7 +18,7 @@ from stickslip.simulation.solve.stages import (
     integral_of_square,
     local_error,
     second_stage,
-    work_of_spring,
+    work_of_force,
 )
 
 from .rig import FAR, MASS, drive, rig, sliding
@@ -89,7 +89,7 @@ def test_work_and_loss_of_a_swing_are_its_integrals():
     pull = lambda t: 0.2 + c_s * (u * t - x(t))  # noqa: E731
     a = tuple(-1e-7 * w**2 * np.sin(w * t + 0.3))
     one = jnp.ones(())
-    work = work_of_spring(tuple(pull(t)), c_s, tuple(x(t)[1:]), tuple(v(t)), a, one, h)
+    work = work_of_force(tuple(pull(t)), c_s, tuple(x(t)[1:]), tuple(v(t)), a, one, h)
     assert work == pytest.approx(quad(lambda t: pull(t) * v(t), 0.0, h, epsrel=1e-13)[0], rel=1e-9)
     square = integral_of_square(tuple(v(t)), a, one, h)
     assert square == pytest.approx(quad(lambda t: v(t) ** 2, 0.0, h, epsrel=1e-13)[0], rel=1e-4)

@@ -99,20 +99,20 @@ def integral_of_square(v: tuple, a: tuple, share: Array, h: Array) -> Array:
     return plain + share * (h * (values + 2.0 * h * rates) - plain)
 
 
-def work_of_spring(
-    pull: tuple, c_s: Array, dx: tuple[Array, Array], v: tuple, a: tuple, share: Array, h: Array
+def work_of_force(
+    force: tuple, stiffness: Array, dx: tuple[Array, Array], v: tuple, a: tuple, share: Array, h: Array
 ) -> Array:
-    """Work (J) of a spring of stiffness ``c_s`` (N/m) whose force is ``pull`` (N) at the start and both stages.
+    """Work (J) of a ``force`` (N; at the start and both stages) that falls by ``stiffness`` (N/m) with displacement.
 
     Where the oscillation is followed the force without the block's displacement is a parabola of time, and the
     displacement that of fifth power through both ends.
     """
-    plain = integral(tuple(f * u for f, u in zip(pull, v, strict=True)), share, h)
-    rise1, rise2 = (f - pull[0] + c_s * way for f, way in zip(pull[1:], dx, strict=True))
+    plain = integral(tuple(f * u for f, u in zip(force, v, strict=True)), share, h)
+    rise1, rise2 = (f - force[0] + stiffness * way for f, way in zip(force[1:], dx, strict=True))
     curve = (rise1 / GAMMA - rise2) / (GAMMA - 1.0)
     way = dx[1]
     # of the displacement over the share s of the step: its integral and that of s times it
     mean = 0.5 * way + 0.1 * h * (v[0] - v[2]) + h * h * (a[0] + a[2]) / 120.0
     moment = (75.0 * way + 8.0 * h * v[0] - 13.0 * h * v[2]) / 210.0 + h * h * (3.0 * a[0] + 4.0 * a[2]) / 840.0
-    along = pull[0] * way - 0.5 * c_s * way**2 + (rise2 - curve) * (way - mean) + curve * (way - 2.0 * moment)
+    along = force[0] * way - 0.5 * stiffness * way**2 + (rise2 - curve) * (way - mean) + curve * (way - 2.0 * moment)
     return jnp.asarray(plain + share * (along - plain))

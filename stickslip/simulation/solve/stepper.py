@@ -23,7 +23,7 @@ import numpy as np
 from jax import Array
 
 from ...physics.contact import Bank
-from ...physics.effects.base import Contact, Motion
+from ...physics.effects.base import BodyForce, Contact, Motion
 from ...physics.model import Forces, Model, State, Work
 from .oscillation import Oscillation, followed, widest
 from .stages import (
@@ -31,11 +31,10 @@ from .stages import (
     D,
     Stage,
     first_stage,
-    integral,
     integral_of_square,
     local_error,
     second_stage,
-    work_of_spring,
+    work_of_force,
 )
 from .tolerance import TINY, Tolerance
 from .trajectory import hermite
@@ -175,13 +174,16 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
                 jnp.where(ok, jnp.maximum(abs(ev) / sv, wide), jnp.inf),
             ),
         )
-        w, block = y0.work, model.block
-        pull, body = (contact.spring_force, f1.spring, f2.spring), (f1.body * v0, f1.body * v1, f2.body * v2)
+        w, block, way = y0.work, model.block, (m1.dx, m2.dx)
+        pull, push = (contact.spring_force, f1.spring, f2.spring), (f1.body, f1.body, f2.body)
+        if any(isinstance(e, BodyForce) for e in model.effects):  # by the equation of motion
+            pushed = model.mass() * a0 - contact.spring_force + jnp.sum(y0.force) + block.damping * v0
+            push = pushed, f1.body, f2.body
         work = Work(
-            w.spring + work_of_spring(pull, block.spring_stiffness, (m1.dx, m2.dx), v, a, share, h),
+            w.spring + work_of_force(pull, block.spring_stiffness, way, v, a, share, h),
             w.friction + f2.dissipated,
             w.viscous + block.damping * integral_of_square(v, a, share, h),
-            w.body + integral(body, share, h) + f2.given,
+            w.body + work_of_force(push, jnp.zeros(()), way, v, a, share, h) + f2.given,
         )
         y1 = eqx.tree_at(lambda y: y.work, y1, work)
         return y1, error, {"y0": y0, "y1": y1}, Step(a2, ~ok), diffrax.RESULTS.successful
