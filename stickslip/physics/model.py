@@ -316,6 +316,25 @@ class Model(Parametrised):
         )
         return State(motion.x, motion.v, force, cap, stiffness, psi, memory, state.work), forces
 
+    def velocity_slope(self, state: State, bank: Bank, contact: Contact, motion: Motion) -> Array:
+        """By how much caps and effects' forces together change with velocity at most, memories apart (N s/m).
+
+        What slides feels the first, not what sticks; it is taken as if all elements did. Zero for most models.
+        """
+
+        def forces(v: Array) -> list[Array]:
+            now = motion._replace(v=v)
+            each = []
+            for e, m in zip(self.effects, state.memory, strict=True):
+                if isinstance(e, Threshold):
+                    each.append(bank.strength * e.strength(m, now, contact))
+                if isinstance(e, BodyForce):
+                    each.append(e.force(m, now, contact))
+            return each
+
+        _, slopes = jax.jvp(forces, (motion.v,), (jnp.ones(()),))
+        return jnp.zeros(()) + sum(jnp.sum(jnp.abs(slope)) for slope in slopes)
+
     def read(self, state: State, motion: Motion, contact_force: Array) -> Array:
         """Displacement (m) that the sensor shows: its effects in the order of their places in the chain."""
         reading = motion.x

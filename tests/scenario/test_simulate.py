@@ -201,9 +201,11 @@ def test_an_output_that_would_not_fit_is_refused():
 
 
 def test_the_default_tolerance_keeps_what_a_scenario_promises():
-    """Recurrence to a thousandth, creep to a nanometre, against a tolerance a hundred times tighter."""
+    """Recurrence to a thousandth, creep to a nanometre, against a tolerance a thousand times tighter."""
     base = make_scenario(rig(contact__bins=128))
-    tight = {f"solver__{key}": getattr(base.file.solver, key) / 100 for key in ("relative", "displacement", "velocity")}
+    tight = {
+        f"solver__{key}": getattr(base.file.solver, key) / 1000 for key in ("relative", "displacement", "velocity")
+    }
     seen, exact = simulate(base), simulate(base.changed(**tight))
     assert exact.attrs["steps"] > 5 * seen.attrs["steps"]
     assert seen["recurrence"].values[1:] == pytest.approx(exact["recurrence"].values[1:], rel=1e-3)

@@ -13,6 +13,7 @@ from jax import Array
 from scipy.interpolate import CubicHermiteSpline
 
 from stickslip.physics.contact import Bank
+from stickslip.physics.effects.direct_effect import DirectEffect
 from stickslip.physics.model import Model, State
 from stickslip.simulation.solve import Tolerance, integrate
 from stickslip.simulation.solve.stepper import ContactStepper
@@ -52,17 +53,21 @@ def fixed_steps(model: Model, state: State, t0: float, t1: float, steps: int) ->
     return float(x), float(v)
 
 
-def oscillator(damping: float = 5.0) -> tuple[Model, State, float, float]:
+def oscillator(damping: float = 5.0, effects: tuple = ()) -> tuple[Model, State, float, float]:
     """A block whose contact never slides; its angular frequency and decay rate (1/s)."""
     stuck = Bank(jnp.array([1e5]), jnp.array([1e3]))
-    model = rig(springs=stuck, load_point=drive((FAR, 0.0)), damping=damping, ratio=1.0)
+    model = rig(springs=stuck, load_point=drive((FAR, 0.0)), damping=damping, ratio=1.0, effects=effects)
     decay = damping / (2.0 * MASS)
     return model, model.rest(v=1e-3), float(np.sqrt(101e3 / MASS - decay**2)), decay
 
 
-def oscillator_errors(steps: np.ndarray, end: float = 0.05) -> np.ndarray:
-    """Error of displacement over its amplitude at ``end`` (s), for numbers of equal steps."""
-    model, state, omega, decay = oscillator()
+def oscillator_errors(steps: np.ndarray, end: float = 0.05, followed: bool = True) -> np.ndarray:
+    """Error of displacement over its amplitude at ``end`` (s), for numbers of equal steps.
+
+    Unless the oscillation is to be ``followed``, what would slide has a law that is too steep for that.
+    """
+    steep = DirectEffect(strengthening=1e-3, cutoff_velocity=1e-8)
+    model, state, omega, decay = oscillator(effects=() if followed else (steep,))
     exact = 1e-3 / omega * np.exp(-decay * end) * np.sin(omega * end)
     return np.array([abs(fixed_steps(model, state, 0.0, end, n)[0] - exact) for n in steps]) * omega / 1e-3
 

@@ -4,14 +4,14 @@ A vector field with kinks handed to a stock solver is an invalid input: the kink
 stops to slide. Here a step is an increment, as in finite elements: position and velocity follow TR-BDF2 (Bank et al.
 1985; L-stable, second order, third-order error estimate of Hosea & Shampine 1996), while contact and effects are
 taken by their own exact or implicit update from the start of the step to each of its two stages. Each stage is a
-scalar equation in the velocity, solved by Newton's method. The path of a step is a parabola: where it turns, and
-where elements stick as the block slows down, is kept without landing on it.
+scalar equation in the velocity, solved by Newton's method. Where the contact holds the block the stages follow its
+oscillation in closed form (:mod:`.stages`). The path of a step is a parabola: where it turns, and where elements stick
+as the block slows down, is kept without landing on it.
 """
 
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -23,16 +23,24 @@ import numpy as np
 from jax import Array
 
 from ...physics.contact import Bank
-from ...physics.effects.base import Contact, Motion
+from ...physics.effects.base import BodyForce, Contact, Motion
 from ...physics.model import Forces, Model, State, Work
-from .tolerance import Tolerance
+from .oscillation import Oscillation, followed, widest
+from .stages import (
+    GAMMA,
+    D,
+    Stage,
+    first_stage,
+    integral_of_square,
+    local_error,
+    second_stage,
+    work_of_force,
+)
+from .tolerance import TINY, Tolerance
 from .trajectory import hermite
 
-GAMMA = 2.0 - math.sqrt(2.0)
-D = GAMMA / 2.0  # weight of the implicit end point in both stages
-W = math.sqrt(2.0) / 4.0  # weight of the start and of the first stage in the second
-# embedded third-order weights minus those of the method
-E0, E1, E2 = (1.0 - W) / 3.0 - W, (3.0 * W + 1.0) / 3.0 - W, D / 3.0 - D
+SHORT = 0.53  # error after which the controller keeps the length of the step
+UNHEARD = 0.3  # of the velocity's amplitude: at most the error of a step that does not follow the oscillation
 
 
 class Increments(diffrax.AbstractTerm):
@@ -122,29 +130,40 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
         tol = self.tolerance
         dh = D * h
         exact = 1e-3 * tol.velocity + 1e-4 * tol.relative * jnp.abs(v0)
+        swing, share = followed(model, bank, y0, contact, a0, t0, h)
 
-        def stage(t: Array, dt: Array, known_dx: Array, known_v: Array, guess: Array) -> tuple:
-            """Solve v = known_v + D h a(v), dx = known_dx + D h v; the path runs from the start of the step."""
-            problem = (model, bank, y0, contact, t, dt, known_dx, known_v, model.lead(t), dh)
+        def stage(t: Array, dt: Array, form: Stage, guess: Array) -> tuple:
+            """Solve for the velocity at the stage; the path runs from the start of the step."""
+            problem = (model, bank, y0, a0, contact, t, dt, form, swing, model.lead(t))
             v, slope, converged, (state, forces, motion) = _root(problem, guess, exact, self.newton_steps)
-            return v, (v - known_v) / dh, state, forces, motion, slope, converged
+            beyond = (v - form.v) / form.into_v
+            a = a0 - swing.stiffness * motion.dx - swing.damping * (v - v0) + beyond
+            return v, a, beyond, state, forces, motion, slope, converged
 
-        tg = t0 + GAMMA * h
-        v1, a1, _, f1, _, _, ok1 = stage(tg, GAMMA * h, dh * v0, v0 + dh * a0, v0)
-        wh = W * h
-        v2, a2, y1, f2, m2, slope, ok2 = stage(t1, h, wh * (v0 + v1), v0 + wh * (a0 + a1), v1)
+        first = first_stage(swing, share, v0, a0, h)
+        v1, a1, n1, _, f1, m1, _, ok1 = stage(t0 + GAMMA * h, GAMMA * h, first, v0 + share * (first.v - v0))
+        second = second_stage(swing, share, (v0, v1), (a0, a1), n1, h)
+        guess = second.v + second.into_v * n1 / GAMMA
+        v2, a2, n2, y1, f2, m2, slope, ok2 = stage(t1, h, second, v1 + share * (guess - v1))
 
-        ex = h * (E0 * v0 + E1 * v1 + E2 * v2)
-        ev = h * (E0 * a0 + E1 * a1 + E2 * a2)
+        v, a = (v0, v1, v2), (a0, a1, a2)
+        ex, ev = local_error(v, a, (n1, n2), share, h)
+        whole = slope * (1.0 + dh * (swing.damping + dh * swing.stiffness))  # with the tangent of the oscillation
+        slope = whole + share * (slope - whole)
         # stiff part of the estimate damped by (1 - D h J)^-1, J the tangent of the second stage
         ex, ev = (ex + dh * ev) / slope, (ev - (slope - 1.0) / dh * ex) / slope
         sx = tol.displacement + tol.relative * m2.path
         sv = tol.velocity + tol.relative * jnp.maximum(abs(v0), abs(v2))
-        held, driving = jnp.maximum(slope - 1.0, 0.0) / dh**2, model.block.spring_stiffness / model.mass()
+        held, driving = jnp.maximum(whole - 1.0, 0.0) / dh**2, model.block.spring_stiffness / model.mass()
         # what rings errs in turns in displacement and velocity; the steps are not to breathe with it
         ex = jnp.sqrt(ex**2 + ev**2 / (held + driving))
         rx, rv = tol.ring(v2, a0, a2, h, held, driving)
         sx, sv = sx + rx, sv + rv
+        # no error would tell of a step so wide that it does not follow what it should
+        rate = jnp.sqrt(swing.stiffness) + TINY
+        rings = jnp.maximum(abs(a0), abs(a2)) / rate + abs(a2 - a0) / (h * rate**2)
+        missed = UNHEARD * rings * jnp.maximum(1.0 / sv, 1.0 / (rate * sx))
+        wide = jnp.where(share > 0.0, jnp.minimum(SHORT * (swing.angle(h) / widest(model)) ** 3, missed), 0.0)
         ok = ok1 & ok2
         error = jax.tree.map(jnp.zeros_like, y0)
         error = eqx.tree_at(
@@ -152,26 +171,22 @@ class ContactStepper(diffrax.AbstractAdaptiveSolver):
             error,
             (
                 jnp.where(ok, ex / sx, jnp.inf),
-                jnp.where(ok, ev / sv, jnp.inf),
+                jnp.where(ok, jnp.maximum(abs(ev) / sv, wide), jnp.inf),
             ),
         )
-        y1 = eqx.tree_at(lambda y: y.work, y1, _work(y0, contact, (v0, v1, v2), (f1, f2), h, model))
+        w, block, way = y0.work, model.block, (m1.dx, m2.dx)
+        pull, push = (contact.spring_force, f1.spring, f2.spring), (f1.body, f1.body, f2.body)
+        if any(isinstance(e, BodyForce) for e in model.effects):  # by the equation of motion
+            pushed = model.mass() * a0 - contact.spring_force + jnp.sum(y0.force) + block.damping * v0
+            push = pushed, f1.body, f2.body
+        work = Work(
+            w.spring + work_of_force(pull, block.spring_stiffness, way, v, a, share, h),
+            w.friction + f2.dissipated,
+            w.viscous + block.damping * integral_of_square(v, a, share, h),
+            w.body + work_of_force(push, jnp.zeros(()), way, v, a, share, h) + f2.given,
+        )
+        y1 = eqx.tree_at(lambda y: y.work, y1, work)
         return y1, error, {"y0": y0, "y1": y1}, Step(a2, ~ok), diffrax.RESULTS.successful
-
-
-def _work(y0: State, contact: Contact, v: tuple, f: tuple, h: Array, model: Model) -> Work:
-    """Energies of the step, by the method's own weights."""
-    v0, v1, v2 = v
-    f1, f2 = f
-
-    def quadrature(p0: Array, p1: Array, p2: Array) -> Array:
-        return h * (W * (p0 + p1) + D * p2)
-
-    spring = quadrature(contact.spring_force * v0, f1.spring * v1, f2.spring * v2)
-    viscous = quadrature(model.block.damping * v0 * v0, f1.viscous * v1, f2.viscous * v2)
-    body = quadrature(f1.body * v0, f1.body * v1, f2.body * v2)
-    w = y0.work
-    return Work(w.spring + spring, w.friction + f2.dissipated, w.viscous + viscous, w.body + body + f2.given)
 
 
 def _path(t: Array, dt: Array, x0: Array, v0: Array, v: Array, dx: Array, lead: Array) -> Motion:
@@ -185,18 +200,20 @@ def _increment(
     model: Model,
     bank: Bank,
     y0: State,
+    a0: Array,
     contact: Contact,
     t: Array,
     dt: Array,
-    known_dx: Array,
-    known_v: Array,
+    form: Stage,
+    swing: Oscillation,
     lead: Array,
-    dh: Array,
 ) -> tuple[Array, tuple[State, Forces, Motion]]:
     """Residual of a stage's equation for the end velocity ``v``, and what the increment then leads to."""
-    motion = _path(t, dt, y0.x, y0.v, v, known_dx + dh * v, lead)
+    dx = form.dx + form.into_dx / form.into_v * (v - form.v)
+    motion = _path(t, dt, y0.x, y0.v, v, dx, lead)
     state, forces = model.advance(y0, bank, contact, motion)
-    return v - known_v - dh * forces.net / model.mass(), (state, forces, motion)
+    beyond = forces.net / model.mass() - a0 + swing.stiffness * dx + swing.damping * (v - y0.v)
+    return v - form.v - form.into_v * beyond, (state, forces, motion)
 
 
 @functools.partial(jax.custom_jvp, nondiff_argnums=(3,))
