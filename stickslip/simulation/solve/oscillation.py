@@ -20,7 +20,7 @@ from ...physics.model import Model, State
 TERMS = 12  # of a power series: what is left out is below 1e-11 of the sum within one radian
 FADES = (1.2, 2.0)  # rad, angles of a step between which the oscillation is followed less and less
 WIDEST, FILTERED = 1.0, 0.5  # rad, angle of a step that follows it; where a sensor filters what happens within the step
-HELD = (0.02, 0.05)  # share of the contact's stiffness that does not slide, from which on the block rings on it
+HELD = (0.25, 0.5)  # share of the contact's stiffness that does not slide, from which on the block rings on it
 STEEP = (1.0, 4.0)  # change of velocity within a step, over itself, by forces that follow it: from there on too stiff
 BLUR = 0.01  # of the way within a step
 
