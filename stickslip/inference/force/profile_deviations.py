@@ -74,6 +74,7 @@ def widened(found: Fit, names: Sequence[str], dispersion: float) -> Fit:
             bent = np.stack([offset / scale, (offset / scale) ** 2], axis=1)
             apart = np.array([p for p, _ in points])
             along = np.linalg.lstsq(likely * bent, likely * apart, rcond=None)[0][0] / scale
+            along[np.diag(found.covariance) == 0.0] = 0.0  # what stands at a bound does not move to either side
             found = replace(found, valleys=(*found.valleys, along * np.sqrt(variance - own)))
     return found
 
