@@ -112,14 +112,14 @@ def test_sliding_friction_that_differs_in_every_event_is_another_drop(plain):
     m, names = data.measurement, [f.name for f in base.free]
     at, ratio = names.index("weakening.drop"), 1.0 - base.values["weakening.drop"]
     z = base.point.z.copy()
-    z[at] = base.free[at].inward(1.0 - ratio * np.exp(0.01))
+    z[at] = base.free[at].inward(1.0 - ratio * np.exp(0.02))
     changes = np.zeros((np.shape(m.cycles.start)[1], len(CHANGES) - 1))
-    changes[:, CHANGES.index("ratio")] = 0.01
+    changes[:, CHANGES.index("ratio")] = 0.02
     _, found, _ = simulated(m, base.problem, base.point, 0, 0, changes)
     _, other, _ = simulated(m, base.problem, replace(base.point, z=z), 0, 0)
     _, as_fitted, _ = simulated(m, base.problem, base.point, 0, 0)
     np.testing.assert_allclose(found, other, rtol=1e-9, atol=1e-15)
-    assert np.nanmax(np.abs(found / as_fitted - 1.0)) > 1e-2  # features differ in their units
+    assert np.abs(found - as_fitted).max() > 1e-3 * np.abs(as_fitted).max()
 
 
 def test_wrong_parameters_show(stronger, confirmed):
